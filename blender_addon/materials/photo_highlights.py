@@ -102,7 +102,9 @@ def reset_view(material: bpy.types.Material) -> None:
         del material[_SEEN]
 
 
-def has_view_changed(material: bpy.types.Material, scene: bpy.types.Scene) -> bool:
+def has_view_changed(
+    material: bpy.types.Material, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
+) -> bool:
     """Return whether light, camera or pose differ from those with which the layer was first shown.
 
     Parameters
@@ -110,7 +112,9 @@ def has_view_changed(material: bpy.types.Material, scene: bpy.types.Scene) -> bo
     material : bpy.types.Material
         A material with the layer; stores the view in which it is first shown.
     scene : bpy.types.Scene
-        The evaluated scene.
+        The scene.
+    depsgraph : bpy.types.Depsgraph
+        The evaluated scene, which has the values of the frame, also while it is rendered.
 
     Returns
     -------
@@ -124,7 +128,7 @@ def has_view_changed(material: bpy.types.Material, scene: bpy.types.Scene) -> bo
     ]
     if not objects:
         return False
-    seen, known = _fingerprint(scene, objects), dict(material.get(_SEEN, {}))
+    seen, known = _fingerprint(scene, objects, depsgraph), dict(material.get(_SEEN, {}))
     if scene.name not in known:
         material[_SEEN] = known | {scene.name: seen}
         return False
@@ -143,15 +147,18 @@ def _output(surface: bpy.types.Node) -> bpy.types.Node | None:
     return None
 
 
-def _fingerprint(scene: bpy.types.Scene, objects: list[Any]) -> str:
-    camera, world = scene.camera, scene.world
-    parts: list[Any] = [_matrix(obj) for obj in objects]
+def _fingerprint(scene: bpy.types.Scene, objects: list[Any], depsgraph: bpy.types.Depsgraph) -> str:
+    camera, world = (
+        block and block.evaluated_get(depsgraph) for block in (scene.camera, scene.world)
+    )
+    parts: list[Any] = [_matrix(obj.evaluated_get(depsgraph)) for obj in objects]
     if camera is not None:
         parts.append(_matrix(camera))
     if camera is not None and camera.type == "CAMERA":  # Blender looks from any object
         lens = camera.data
         parts += [lens.type, lens.lens, lens.ortho_scale, lens.shift_x, lens.shift_y]
-    for lamp in (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render):
+    lamps = [obj.evaluated_get(depsgraph) for obj in scene.objects if obj.type == "LIGHT"]
+    for lamp in (one for one in lamps if not one.hide_render):
         light = lamp.data
         parts += [_matrix(lamp), light.type, light.energy, list(light.color)]
     if world is not None and world.node_tree is not None:

@@ -1,10 +1,10 @@
 """Handlers that follow edits, by a slider, a script, undo or the node editor.
 
-After each update of the scene, edits are written into the material (`material_edits`), and
-highlights of the photo that are no longer valid for the view are turned off
-(`photo_highlights`). Baking waits until no slider has moved for a moment, and computes the
-colours in a thread, which a later edit stops; without a window, and before a file is saved or
-exported, it happens at once.
+After each update of the scene, edits are written into the material (`material_edits`). After it,
+and after each change of the frame, highlights of the photo that are no longer valid for the view
+are turned off (`photo_highlights`). Baking waits until no slider has moved for a moment, and
+computes the colours in a thread, which a later edit stops; without a window, and before a file is
+saved or exported, it happens at once.
 
 glTF's exporter asks for `prepare_export` and `finish_export` through the functions of the package
 that are named after its interface.
@@ -43,6 +43,7 @@ _HIDDEN_FOR_EXPORT = "isc_hidden_for_export"
 def add_handlers() -> None:
     """Follow edits from now on."""
     bpy.app.handlers.depsgraph_update_post.append(_after_update)
+    bpy.app.handlers.frame_change_post.append(_after_frame_change)
     bpy.app.handlers.save_pre.append(_before_saving)
     for before in (bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre):
         before.append(_before_undo)
@@ -57,6 +58,7 @@ def remove_handlers() -> None:
     for before in (bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre):
         before.remove(_before_undo)
     bpy.app.handlers.save_pre.remove(_before_saving)
+    bpy.app.handlers.frame_change_post.remove(_after_frame_change)
     bpy.app.handlers.depsgraph_update_post.remove(_after_update)
     _stop_bakes()
     for timer in (_bake_when_idle, _clear_status):
@@ -136,13 +138,22 @@ def _after_update(scene: Any, depsgraph: Any) -> None:
         for material in _materials():
             write_edits(material)
     if any(depsgraph.id_type_updated(kind) for kind in _VIEW_KINDS):
-        for material in _materials():
-            if shows_highlights(material) and has_view_changed(material, scene):
-                hide_highlights(material)
-                write_edits(material)
-                _show_status(
-                    f"{material.name}: photo highlights turned off, because the view changed"
-                )
+        _hide_outdated_highlights(scene, depsgraph)
+
+
+@persistent
+def _after_frame_change(scene: Any, depsgraph: Any) -> None:
+    # A render in the background of a window reads the materials at the same time.
+    if not bpy.app.is_job_running("RENDER") or scene.render.use_lock_interface:
+        _hide_outdated_highlights(scene, depsgraph)
+
+
+def _hide_outdated_highlights(scene: Any, depsgraph: Any) -> None:
+    for material in _materials():
+        if shows_highlights(material) and has_view_changed(material, scene, depsgraph):
+            hide_highlights(material)
+            write_edits(material)
+            _show_status(f"{material.name}: photo highlights turned off, because the view changed")
 
 
 @persistent

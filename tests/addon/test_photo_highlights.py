@@ -117,6 +117,24 @@ def test_a_new_light_hides_the_layer(built: BuiltObject) -> None:
     assert not shows_highlights(built.material)
 
 
+@pytest.mark.parametrize("moved", ["object", "camera", "lamp"])
+def test_an_animation_hides_the_layer(built: BuiltObject, moved: str) -> None:
+    """At frames at which nothing has moved yet it stays."""
+    one = {"object": built.object, "camera": built.camera, "lamp": bpy.data.objects["lamp"]}[moved]
+    assert one is not None
+    for frame, angle in ((5, 1.0), (4, 0.0), (1, 0.0)):
+        one.rotation_mode, one.rotation_euler[2] = "XYZ", angle
+        one.keyframe_insert("rotation_euler", index=2, frame=frame)
+    built.scene.frame_set(1)
+    bpy.ops.isc.photo_highlights(show=True)
+    bpy.context.view_layer.update()
+    assert shows_highlights(built.material)
+    built.scene.frame_set(4)
+    assert shows_highlights(built.material)
+    built.scene.frame_set(5)
+    assert not shows_highlights(built.material)
+
+
 @pytest.mark.slow
 def test_with_the_layer_the_object_looks_as_in_the_photo(
     addon: Any, bump_folder: Path, tmp_path: Path
