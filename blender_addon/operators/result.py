@@ -12,6 +12,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from isc_core.errors import InputError
 
+from ..datablocks.provenance import find_tagged
 from ..datablocks.staging import run_to_end
 from ..files.result_arrays import DESCRIPTION
 from ..runs.active_run import require_no_active_run
@@ -26,8 +27,9 @@ from ..runs.request import (
 )
 from ..runs.run_steps import import_steps, read_and_prepare
 from ..runs.worker_run import ImportSteps, RunOutput, WorkerRun, remove_folder
-from ..scene.build import StagedObject
+from ..scene.build import StagedObject, key_of
 from ..scene.built_object import BuiltObject, find_built
+from ..scene.copies import OBJECT
 from ..scene.objects import discard, place_objects, stage_objects
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .modal import WorkerOperator
@@ -82,7 +84,9 @@ def build_in_steps(
         raise InputError(error_line(error)) from error
     finally:
         discard(_staged.pop(folder))
-    built = find_built(bpy.context.object)
+    # It is not active if its collection is excluded.
+    key = key_of(prepared[0], find_by_full_name(bpy.data.images, request.image))
+    built = find_built(find_tagged(bpy.data.objects, key, OBJECT))
     if built is None:
         return "the object is in the scene"
     what = built.object.name if len(prepared) == 1 else f"{len(prepared)} objects"

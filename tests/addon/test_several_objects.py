@@ -21,6 +21,7 @@ from blender_addon.operators import result  # noqa: E402
 from blender_addon.operators.modal import advance_run  # noqa: E402
 from blender_addon.runs.active_run import begin_run  # noqa: E402
 from blender_addon.runs.request import DecomposeRequest, request_from_settings  # noqa: E402
+from blender_addon.runs.worker_run import RunOutput  # noqa: E402
 from blender_addon.scene.built_object import find_built  # noqa: E402
 from blender_addon.scene.objects import place_objects, prepare_objects, stage_objects  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
@@ -359,3 +360,14 @@ def test_the_active_object_stays_active_when_all_are_updated(addon: Any, tmp_pat
     addon.context.view_layer.objects.active = addon.data.objects["pair 2"]
     addon.ops.isc.build_result(directory=str(tmp_path), request=request.to_json())
     assert addon.context.object.name == "pair 2"
+
+
+def test_the_message_names_an_object_in_an_excluded_collection(addon: Any, tmp_path: Path) -> None:
+    results = several_results(tmp_path)
+    request = DecomposeRequest(build=BuildOptions(own_scene=False))
+    output = RunOutput(results[0].folder)
+    assert result.build_as_undo_step(addon.context, output, request).startswith("bump created")
+    entries = addon.context.view_layer.layer_collection.children
+    entries["bump"].exclude = True
+    assert result.build_as_undo_step(addon.context, output, request) == "bump updated"
+    assert entries["bump"].exclude
