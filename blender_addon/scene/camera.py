@@ -41,8 +41,8 @@ def ensure_camera(
     size_metres : float
         Longer side of the object.
     transform : Matrix, optional
-        Transform of the object, of which location and rotation are used; at the world origin if
-        None.
+        Transform of the object; at the world origin if None. Of an uneven scale, the one across the
+        view counts.
     photo_frame : bool, optional
         Whether the frame is the photo's instead of that of the maps.
 
@@ -60,8 +60,10 @@ def ensure_camera(
         link_object(camera, collection)
     frame = _photo_frame(result) if photo_frame else result.size
     fit = _fit_orthographic if result.focal_length is None else _fit_pinhole
-    position = fit(camera.data, result, metres_per_pixel(result, size_metres), frame)
-    place = Matrix() if transform is None else Matrix.LocRotScale(*transform.decompose()[:2], None)
+    location, rotation, scale = (transform or Matrix()).decompose()
+    across = abs(scale.x * scale.z) ** 0.5 or 1.0
+    position = fit(camera.data, result, metres_per_pixel(result, size_metres) * across, frame)
+    place = Matrix.LocRotScale(location, rotation, None)
     # Not its basis: users may have given it a parent.
     camera.matrix_world = (
         place @ Matrix.Translation(position) @ Matrix.Rotation(0.5 * np.pi, 4, "X")

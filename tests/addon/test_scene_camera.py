@@ -49,6 +49,7 @@ def test_the_camera_follows_an_object_that_was_moved(
     built = build(result)
     before = render(built.scene, tmp_path)["Diffuse Color"]
     built.object.location, built.object.rotation_euler = (1.0, -2.0, 0.5), (0.3, 0.2, 1.0)
+    built.object.scale = (1.5, 1.5, 1.5)
     built = build(result)
     assert tuple(built.object.location) == pytest.approx((1.0, -2.0, 0.5)), (
         "what people moved stays where it is"

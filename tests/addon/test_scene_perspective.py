@@ -65,6 +65,7 @@ def test_each_vertex_is_seen_at_its_pixel(blender: Any, result: ResultArrays, mo
     built = build(result, size_metres=0.7)
     if moved:
         built.object.location, built.object.rotation_euler = (1.0, -2.0, 0.5), (0.3, 0.2, 1.0)
+        built.object.scale = (1.5, 1.5, 1.5)
         built = build(result, size_metres=0.7)
     assert built.camera.data.type == "PERSP"
     vertices = evaluated_vertices(built)
