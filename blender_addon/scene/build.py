@@ -28,6 +28,7 @@ from ..datablocks.provenance import (
     SOURCE_IMAGE,
     datablock_name,
     find_tagged,
+    is_isc_datablock,
     photo_hash,
     require_local,
     tag,
@@ -477,6 +478,8 @@ def _set_scene(built: BuiltObject, options: BuildOptions, result: ResultArrays) 
     """
     scene, own = built.scene, options.own_scene
     if options.set_world or (own and scene.world is None):
+        if scene.world is not None and not is_isc_datablock(scene.world):
+            scene.world.use_fake_user = True  # else it would not be saved
         scene.world = built.world
     if options.set_camera or (own and scene.camera is None):
         scene.camera = built.camera

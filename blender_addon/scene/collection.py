@@ -30,7 +30,7 @@ def ensure_collection(
     Returns
     -------
     bpy.types.Collection
-        The collection.
+        The collection; for a new object, view layers include it.
     """
     collection = find_tagged(bpy.data.collections, key, "collection")
     if collection is None:
@@ -39,7 +39,19 @@ def ensure_collection(
         return collection
     if collection not in set(scene.collection.children_recursive):
         scene.collection.children.link(collection)
+    if obj is None and not is_included(collection, scene):
+        _include(collection, scene)
     return collection
+
+
+def _include(collection: bpy.types.Collection, scene: bpy.types.Scene) -> None:
+    """Check a collection in the view layers of a scene; what is in it stays unchecked."""
+    for layer in scene.view_layers:
+        entry = layer.layer_collection and find_layer_collection(layer.layer_collection, collection)
+        if entry:
+            entry.exclude = False
+            for child in entry.children:
+                child.exclude = True
 
 
 def ensure_scene(

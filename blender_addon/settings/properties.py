@@ -271,7 +271,9 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     )
     set_world: BoolProperty(
         name="World",
-        description="Replace the scene's world with the recovered light",
+        description=(
+            "Replace the scene's world with the recovered light; the world stays in the file"
+        ),
         default=False,
     )
     set_camera: BoolProperty(

@@ -295,6 +295,36 @@ def test_each_option_changes_one_setting_of_the_scene(
     assert {name for name, changed in CHANGES.items() if changed(scene, built)} == {chosen}
 
 
+def test_a_world_that_is_replaced_is_saved(
+    blender: Any, result: ResultArrays, tmp_path: Path
+) -> None:
+    scene = blender.context.scene
+    scene.world = blender.data.worlds.new("studio")
+    build(result, own_scene=False)
+    assert not scene.world.use_fake_user
+    for _ in range(2):
+        built = build(result, own_scene=False, set_world=True)
+        assert scene.world == built.world and not built.world.use_fake_user
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    blender.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    assert "studio" in blender.data.worlds
+
+
+def test_a_new_object_is_seen_although_its_former_collection_is_excluded(
+    blender: Any, result: ResultArrays
+) -> None:
+    built = build(result, own_scene=False)
+    entries = blender.context.view_layer.layer_collection.children
+    entries[built.collection.name].exclude = True
+    assert build(result, own_scene=False).object.name not in blender.context.view_layer.objects
+    assert entries[built.collection.name].exclude, "an update keeps what the user has set"
+    blender.data.objects.remove(built.object)
+    built = build(result, own_scene=False)
+    assert built.object.name in blender.context.view_layer.objects
+    (part,) = entries[built.collection.name].children
+    assert part.exclude, "the photo's sun does not shine"
+
+
 def test_a_scene_can_be_chosen(blender: Any, result: ResultArrays) -> None:
     other = blender.data.scenes.new("other")
     assert build(result, scene=other, own_scene=False).object.name in other.objects
