@@ -55,6 +55,7 @@ from .collection import (
     ensure_scene,
     is_in_scene,
     link_object,
+    use_part,
     use_standard_view,
 )
 from .copies import (
@@ -263,7 +264,7 @@ def _place(
     if options.own_scene:
         scene = ensure_scene(key, scene, existing)
     collection = ensure_collection(key, scene, existing)
-    light = _light_before(existing, options)
+    light, had_sun = _light_before(existing, options), _stored_option(existing, "sun", False)
     images = {
         role: replace_image(image, key, role)
         for role in prepared.files
@@ -303,6 +304,8 @@ def _place(
     restore_light(obj, light, scene)
     keep_sun = light.ambient is not None
     camera = _ensure_camera_and_light(key, collection, obj, result, options, scene, keep_sun)
+    if had_sun and not options.sun and scene.camera != camera:
+        _leave_part(key, scene)
     photo = photo or images.get(ImageRole.PHOTO)
     if camera is not None and photo is not None:
         set_background_photo(camera, photo)
@@ -331,11 +334,22 @@ def _ensure_materials(
 
 def _light_before(existing: bpy.types.Object | None, options: BuildOptions) -> ShownLight:
     """The light of an object that is updated, unless another one is requested than before."""
-    if existing is not None:
-        before = json.loads(existing.get("isc_options", "{}"))
-        if before.get("sun", options.sun) == options.sun:
-            return shown_light(existing)
+    if existing is not None and _stored_option(existing, "sun", options.sun) == options.sun:
+        return shown_light(existing)
     return ShownLight(options.sun)
+
+
+def _stored_option(obj: bpy.types.Object | None, name: str, default: bool) -> bool:
+    """An option with which an object was built last."""
+    stored = {} if obj is None else json.loads(obj.get("isc_options", "{}"))
+    return bool(stored.get(name, default))
+
+
+def _leave_part(key: str, scene: bpy.types.Scene) -> None:
+    """Exclude the photo's light and camera, which were included for the sun."""
+    part = find_tagged(bpy.data.collections, key, LIGHT_AND_CAMERA)
+    if part is not None:
+        use_part(part, scene, False)
 
 
 def _lamps(result: ResultArrays) -> tuple[np.ndarray, np.ndarray]:

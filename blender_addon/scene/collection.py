@@ -123,13 +123,28 @@ def ensure_optional_part(
         part = tag(bpy.data.collections.new(datablock_name(key, role)), key, role)
         collection.children.link(part)
     if is_new or shown:
-        for layer in scene.view_layers:
-            if layer.layer_collection is None:  # of a scene that was never shown (Blender 5.3)
-                layer.update()
-            entry = find_layer_collection(layer.layer_collection, part)
-            if entry is not None:
-                entry.exclude = not shown
+        use_part(part, scene, shown)
     return part
+
+
+def use_part(part: bpy.types.Collection, scene: bpy.types.Scene, shown: bool) -> None:
+    """Set whether the view layers of a scene use a collection.
+
+    Parameters
+    ----------
+    part : bpy.types.Collection
+        The collection.
+    scene : bpy.types.Scene
+        The scene.
+    shown : bool
+        Whether they include it.
+    """
+    for layer in scene.view_layers:
+        if layer.layer_collection is None:  # of a scene that was never shown (Blender 5.3)
+            layer.update()
+        entry = find_layer_collection(layer.layer_collection, part)
+        if entry is not None:
+            entry.exclude = not shown
 
 
 def find_layer_collection(

@@ -222,3 +222,16 @@ def test_lamps_leave_the_recovered_shading(
     seen, where = lit(build(with_lamps(result, 2)), result, tmp_path)
     wanted = result.shading[where] / result.reflectance_scale
     np.testing.assert_allclose((seen / wanted).mean(0), 1, atol=0.002)
+
+
+def test_without_estimated_sun_an_update_takes_it_out_of_the_scene(
+    blender: Any, bump_folder: Path
+) -> None:
+    result, layer = read_result(bump_folder), blender.context.view_layer
+    for sun in (False, True, False, True):
+        built = build(result, own_scene=False, sun=sun)
+        layer.update()
+        assert ("SUN" in [obj.data.type for obj in layer.objects if obj.type == "LIGHT"]) == sun
+    built.scene.camera = built.camera
+    build(result, own_scene=False)
+    assert built.camera.name in layer.objects, "the user looks through it"
