@@ -338,6 +338,7 @@ def _input_json(photo: Photo, corner: tuple[int, int], name: str) -> dict[str, o
         "colour_profile": source.colour_profile,
         "reading_notes": [{"kind": one.kind.value, "value": one.value} for one in source.notes],
         "mask_from": source.mask_from,
+        **({"object": source.object_number} if source.object_number else {}),
         **_marks_json(photo, corner),
         **({} if source.confidence is None else {"mask_confidence": round(source.confidence, 4)}),
     }

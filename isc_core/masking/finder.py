@@ -190,6 +190,7 @@ def photos_of_each_object(
     return [
         replace(
             one,
+            original=replace(one.original, object_number=number),
             problem=mask_problem(one.mask, f"{name}: the mask of object {number}")
             or constant_problem(raster.values, inside, one.mask),
         )

@@ -39,6 +39,8 @@ class PhotoSource:
         The metadata give a focal length, but for a frame of another aspect ratio: it is not valid.
     confidence : float or None
         Of a mask that was found automatically or by hints, see `FoundMask`.
+    object_number : int
+        Of one of several objects of the photo, from 1; 0 if the photo is of one object.
     """
 
     sha256: str
@@ -50,6 +52,7 @@ class PhotoSource:
     notes: tuple[ReadingNote, ...] = ()
     cropped: bool = False
     confidence: float | None = None
+    object_number: int = 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -341,6 +341,8 @@ def _title(d: Decomposition, shape: tuple[int, ...]) -> tuple[str, str]:
     given, settings = d.provenance.input, d.provenance.settings
     diagnostics = d.provenance.diagnostics
     name = PurePath(str(given.get("name", ""))).name or "Decomposition"
+    if given.get("object"):
+        name += f", object {given['object']}"
     parts = [f"{shape[1]} x {shape[0]} px"]
     parts += [
         str(settings[key]) for key in ("model", "separator", "illumination") if settings.get(key)

@@ -115,6 +115,7 @@ def test_a_failing_object_does_not_stop_the_others(
     assert isc("decompose", photo, "--each", *NAIVE, "-q", "-o", tmp_path / "all") == 0
     kept, alone = (load(folder / "2") for folder in (out, tmp_path / "all"))
     assert np.array_equal(kept.reflectance, alone.reflectance)
+    assert kept.provenance.input["object"] == 2
     assert isc(*words, "--progress", "json") == 1
     last = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert last["event"] == "failed" and last["code"] == 1 and "object 1 of 2: " in last["message"]

@@ -334,8 +334,8 @@ def test_a_comparison_without_truth_shows_the_confidence(scene: Decomposition) -
     )
 
 
-def drawn_subtitle(d: Decomposition) -> str:
-    """The second line of text that the contact sheet draws."""
+def drawn_text(d: Decomposition) -> list[str]:
+    """The lines of text that the contact sheet draws: title, subtitle, and so on."""
     drawn: list[str] = []
     text = ImageDraw.ImageDraw.text
 
@@ -346,7 +346,11 @@ def drawn_subtitle(d: Decomposition) -> str:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ImageDraw.ImageDraw, "text", recorded)
         contact_sheet(d)
-    return drawn[1]
+    return drawn
+
+
+def drawn_subtitle(d: Decomposition) -> str:
+    return drawn_text(d)[1]
 
 
 @pytest.mark.slow
@@ -381,3 +385,11 @@ def test_the_title_says_that_clipping_hides_the_highlights() -> None:
         lobe = LobeDiagnostics(status, LobeFitOutcome.NO_SPECULAR)
         provenance = replace(d.provenance, diagnostics=Diagnostics(lobe=lobe))
         assert drawn_subtitle(replace(d, brdf=nothing, provenance=provenance)).endswith(said)
+
+
+def test_the_title_has_the_number_of_one_of_several_objects() -> None:
+    d = ball()
+    named = d.provenance.input | {"name": "shelf.png"}
+    for numbered, title in ((named, "shelf.png"), (named | {"object": 2}, "shelf.png, object 2")):
+        about = replace(d, provenance=replace(d.provenance, input=numbered))
+        assert drawn_text(about)[0] == title
