@@ -33,7 +33,7 @@ from .build import StagedObject, key_of, place_object, require_placeable, stage_
 from .built_object import LIGHT_OF, BuiltObject
 from .camera import eye_of
 from .placement import world_matrix
-from .preparation import BuildOptions, PreparedObject, prepare
+from .preparation import BuildOptions, PreparedObject, fit_size, prepare
 
 _CONSTANT = 0.5 / np.sqrt(np.pi)  # the first spherical harmonic
 _LEAST = 1e-9
@@ -81,10 +81,11 @@ def prepare_objects(
         if index != first:
             none: dict[str, Any] = dict.fromkeys(_SHARED, False)
             own = replace(own, own_shadows=shadows, **none)
-        prepared = prepare(relit[index], own, with_photo=with_photo and index == first)
+        shows_photo = with_photo and index == first
+        prepared = prepare(relit[index], own, with_photo=shows_photo, fit=False)
         offset = offset_between(results[first], results[index], step)
         made.append(replace(prepared, offset=offset))
-    return made
+    return fit_size(made, options.size_metres)
 
 
 def offset_between(

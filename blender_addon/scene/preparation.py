@@ -3,7 +3,7 @@
 Nothing here accesses a datablock, so it may run in another thread while the window is used.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -113,7 +113,7 @@ class PreparedObject:
     result : ResultArrays
         The result.
     options : BuildOptions
-        What will be built from it.
+        What will be built from it; before a pinhole camera, the size is that of its middle.
     mesh : MeshArrays
         The mesh.
     checksum : str
@@ -136,7 +136,7 @@ class PreparedObject:
 
 
 def prepare(
-    result: ResultArrays, options: BuildOptions, *, with_photo: bool = False
+    result: ResultArrays, options: BuildOptions, *, with_photo: bool = False, fit: bool = True
 ) -> PreparedObject:
     """Do the slow part of building an object.
 
@@ -148,6 +148,8 @@ def prepare(
         What will be built from it.
     with_photo : bool, optional
         Whether the masked photo of the result becomes an image.
+    fit : bool, optional
+        Whether `fit_size` gives the object its size; otherwise its middle has it.
 
     Returns
     -------
@@ -170,7 +172,46 @@ def prepare(
         files = {role: file.result() for role, file in encoded.items()} | colored.result()
     if normal_map is not None:
         files[ImageRole.NORMAL_MAP] = normal_map
-    return PreparedObject(result, options, mesh, checksum, files, specular)
+    prepared = PreparedObject(result, options, mesh, checksum, files, specular)
+    return fit_size([prepared], options.size_metres)[0] if fit else prepared
+
+
+def fit_size(prepared: Sequence[PreparedObject], size_metres: float) -> list[PreparedObject]:
+    """Scale objects before a pinhole camera, whose outlines and backs are farther away than their
+    middles, and therefore larger than these.
+
+    Parameters
+    ----------
+    prepared : sequence of PreparedObject
+        One object, or the objects of one photo.
+    size_metres : float
+        Longer side of the largest one.
+
+    Returns
+    -------
+    list of PreparedObject
+        Scaled by one factor; unchanged without a pinhole camera, and where the shape is the
+        result's own, whose middle the size is measured by.
+    """
+    if any(
+        one.result.eye is None or one.options.displacement or not one.options.back
+        for one in prepared
+    ):
+        return list(prepared)
+    sides = [np.ptp(one.mesh.positions.reshape(-1, 3), axis=0)[[0, 2]].max() for one in prepared]
+    return [_scaled(one, size_metres / float(max(sides))) for one in prepared]
+
+
+def _scaled(prepared: PreparedObject, factor: float) -> PreparedObject:
+    mesh = replace(prepared.mesh, positions=prepared.mesh.positions * np.float32(factor))
+    x, y, z = prepared.offset
+    return replace(
+        prepared,
+        options=replace(prepared.options, size_metres=prepared.options.size_metres * factor),
+        mesh=mesh,
+        checksum=mesh_checksum(mesh),
+        offset=(factor * x, factor * y, factor * z),
+    )
 
 
 def _shape(result: ResultArrays, options: BuildOptions) -> tuple[MeshArrays, str, ImageFile | None]:

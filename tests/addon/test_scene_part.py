@@ -107,11 +107,14 @@ def test_the_scene_is_that_of_the_whole_frame(
     assert part.mask.size < 0.5 * FRAME[0] * FRAME[1]
     whole = of_whole_frame(part)
     near, far = build(part, **options, name="part"), build(whole, **options, name="whole")
+    # Before a camera, a solid is as large as asked, and its back differs slightly in another frame.
+    rtol = 1e-3 if options.get("back") else 1e-6
     np.testing.assert_allclose(
-        np.array(near.camera.matrix_world), np.array(far.camera.matrix_world), atol=1e-6
+        np.array(near.camera.matrix_world), np.array(far.camera.matrix_world), rtol, atol=1e-6
     )
     for value in ("lens", "ortho_scale", "shift_x", "shift_y", "clip_start", "clip_end"):
-        assert getattr(near.camera.data, value) == pytest.approx(getattr(far.camera.data, value))
+        expected = getattr(far.camera.data, value)
+        assert getattr(near.camera.data, value) == pytest.approx(expected, rel=rtol)
     images = [render(built.scene, tmp_path)["Combined"] for built in (near, far)]
     assert images[0].shape[:2] == FRAME
     seen = [image[..., 3] > 0.5 for image in images]

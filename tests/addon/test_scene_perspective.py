@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
+from blender_addon.scene.hand_edits import is_edited_by_hand
 from isc_core.errors import InputError
 from isc_core.photo.camera import Camera
 from isc_core.result_files.arrays_file import mesh_of, write_arrays
@@ -73,10 +74,18 @@ def test_each_vertex_is_seen_at_its_pixel(blender: Any, result: ResultArrays, mo
     assert np.abs(off).max() < 0.01
 
 
-def test_the_longer_side_has_the_given_size(blender: Any, result: ResultArrays) -> None:
-    """Although the outline of the object is farther away than its middle."""
-    longer = max(np.ptp(evaluated_vertices(build(result, size_metres=0.7)), axis=0)[[0, 2]])
-    assert longer == pytest.approx(0.7, rel=0.03)  # and one pixel
+@pytest.mark.parametrize("back", ["", "open", "flat", "rounded", "mirrored"])
+def test_the_longer_side_has_the_given_size(blender: Any, result: ResultArrays, back: str) -> None:
+    """Although the outline and the back of the object are farther away than its middle."""
+    for _ in range(2):
+        built = build(result, size_metres=0.7, back=back)
+        vertices = evaluated_vertices(built)
+        assert max(np.ptp(vertices, axis=0)[[0, 2]]) == pytest.approx(
+            0.7, rel=1e-4 if back else 0.03
+        )
+        assert not is_edited_by_hand(built.object)
+    front = seen_pixels(built, vertices)[vertices[:, 1].argmin()]
+    assert result.mask[tuple(np.rint(front).astype(int))]
 
 
 def test_a_displaced_grid_is_seen_alike_at_any_strength(blender: Any, result: ResultArrays) -> None:

@@ -307,6 +307,20 @@ def test_one_pinhole_camera_sees_each_object_where_the_photo_does(
     for one, seen in zip(built, results, strict=True):
         off = seen_pixels(replace(one, camera=built[0].camera), evaluated_vertices(one))
         assert np.abs(off - seen.vertex_pixel).max() < 0.01
+    options = BuildOptions(name="solids", each=True, back="flat", size_metres=0.5)
+    solids = place_objects(run_to_end(stage_objects(prepare_objects(results, options))))
+    corners = [evaluated_vertices(one) for one in solids]
+    assert max(np.ptp(one, axis=0)[[0, 2]].max() for one in corners) == pytest.approx(0.5, rel=1e-4)
+    for solid, points, first in zip(solids, corners, built, strict=True):
+        pixels, before = (
+            seen_pixels(replace(one, camera=camera), vertices)
+            for one, camera, vertices in (
+                (solid, solids[0].camera, points),
+                (first, built[0].camera, evaluated_vertices(first)),
+            )
+        )
+        assert np.abs(pixels.max(0) - before.max(0)).max() < 2
+        assert np.abs(pixels.min(0) - before.min(0)).max() < 2
 
 
 def test_staging_does_not_need_the_photo_again(blender: Any, tmp_path: Path) -> None:
