@@ -37,7 +37,7 @@ from .height_bumps import HeightBumps
 from .held_out import held_out_blocks, pixels_of
 from .working_scale import WorkingScale
 
-_SPACINGS, _SLOPES = (0.03, 0.12), (0.2, 0.2)  # spacings: fractions of the object's longer side
+_SPACINGS, _SLOPES = (0.03, 0.12), (0.1, 0.1)  # spacings: fractions of the object's longer side
 _MIN_SPACING = 2.0  # pixels
 _BLOCKS, _SHARE = (2, 8), 5  # sides of a block, pixels; one in this many blocks is held out
 _BRIGHT, _ACROSS = 0.3, 4  # of the peak; blocks across the bright area

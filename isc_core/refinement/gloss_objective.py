@@ -5,7 +5,8 @@ normals n of these slopes, the gloss is G = sum_k E_k f(n, l_k; alpha), f the GG
 cosine. A separator returns only light above an unknown level b, so s ~ max(G - b, 0), softened:
 
     F = w sum_p 2 (sqrt(1 + r_p^2) - 1) + (|u|^2 + (log(alpha / alpha_0) / .28)^2
-        + |l_0 - l*|^2 / c^2 + (max(log(sum E / E*), 0) / .3)^2 + (log(b / b_0) / .5)^2) / 2,
+        + (max(log(sum E / E*), 0) / .3)^2 + (log(b / b_0) / .5)^2) / 2
+        + log(1 + |l_0 - l*|^2 / (2 c^2)),
     r = (max(G - b, 0) - s) / sqrt((.03 P)^2 + (.15 s)^2)
 
 P is the peak of s, l* the light of the initial lobe, alpha_0 its roughness, E* its irradiance
@@ -36,7 +37,7 @@ from .height_bumps import HeightBumps
 ROUGHNESS_SPREAD = 0.28  # of log alpha, from `lobe_fitting.recovered`
 _WEIGHT = 0.05
 _FLOOR, _RELATIVE = 0.03, 0.15
-_CONE = 0.26  # radians, 15 degrees
+_CONE = 0.05  # radians, 3 degrees; a heavy tail, as one of four predicted lamps is over 10 off
 _TOO_BRIGHT, _LEVEL_SPREAD = 0.3, 0.5
 _LEVEL = 0.02  # b_0 over P
 _SOFT = 0.02  # of P
@@ -302,11 +303,12 @@ class GlossObjective:
         to_strength += bright / _TOO_BRIGHT * strengths / strengths.sum()
         unit = gloss.units[0]
         turn = (unit - data.direction) / _CONE
-        along = turn / _CONE
+        tail = 1 + 0.5 * float((turn * turn).sum())
+        along = turn / (_CONE * tail)
         to_direction[0] += (along - (along * unit).sum() * unit) / np.linalg.norm(
             gloss.directions[0]
         )
-        return 0.5 * float(rough**2 + level**2 + bright**2 + (turn * turn).sum())
+        return 0.5 * float(rough**2 + level**2 + bright**2) + float(np.log(tail))
 
     def _parts(
         self, gradient: np.ndarray, count: int
