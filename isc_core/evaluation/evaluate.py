@@ -287,14 +287,13 @@ def evaluate(
         raise InputError("nothing to evaluate: name at least one object and one illumination")
     for light, name in jobs:
         check_request(root, name, light, input)
-    truths = [load_object(root, name, light, input) for light, name in jobs]
-    for truth in truths:
-        require_truth(truth)
+    for light, name in jobs:  # read again below: a large set does not fit in memory
+        require_truth(load_object(root, name, light, input))
     results = []
     for done, (light, name) in enumerate(jobs):
         part = monitor.part(done / len(jobs), (done + 1) / len(jobs))
         part.report(f"{name}, {light}", 0.0)
-        results.append(_run(truths.pop(0), runner, part))
+        results.append(_run(load_object(root, name, light, input), runner, part))
     monitor.report("evaluated", 1.0)
     return EvaluationReport(model, input, tuple(results), protocol)
 

@@ -263,19 +263,6 @@ def test_a_glossy_set_is_evaluated_once_under_its_own_light(
     assert found.illuminations == (light.partition("-")[0],) and len(found.results) == 2
 
 
-def test_each_object_is_read_once(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was checked is what is scored, even if the files change during the runs."""
-    read: list[str] = []
-
-    def counted(where: Path, name: str, light: str, kind: str) -> MitBerkeleyObject:
-        read.append(f"{name}, {light}")
-        return load_object(where, name, light, kind)
-
-    monkeypatch.setattr("isc_core.evaluation.evaluate.load_object", counted)
-    evaluate(root, model="naive", runner=naive)
-    assert len(read) == len(set(read)) == 4
-
-
 def test_bad_names_are_found_before_the_first_run(root: Path) -> None:
     def never(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
         raise AssertionError("must not run")
