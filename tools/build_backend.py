@@ -55,7 +55,6 @@ PACKAGES = {
 LEFT_OUT = (
     "benchmarks/batch",
     "benchmarks/blender",
-    "benchmarks/bootstrap.py",
     "benchmarks/decomposition",
     "benchmarks/detail",
     "benchmarks/refinement/closed_loop.py",

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..datablocks.provenance import KEY, PHOTO_HASH, ROLE, find_tagged, is_isc_datablock
+from ..datablocks.provenance import KEY, ROLE, find_tagged, is_isc_datablock
 from .collection import is_in_scene
-from .copies import COPY, OBJECT, find_material
+from .copies import COPY, OBJECT, are_of_one_photo, find_material
 from .world import world_of
 
 LIGHT_OF = "isc_light_of"  # of an object: the key of the object of its photo that has the light
@@ -113,7 +113,7 @@ def light_owner(built: BuiltObject) -> BuiltObject:
     owner = find_tagged(bpy.data.objects, obj.get(LIGHT_OF, ""), OBJECT)
     if owner is None or built.scene is None or not is_in_scene(owner, built.scene):
         return built
-    if owner.get(PHOTO_HASH) != obj.get(PHOTO_HASH):  # of a file to which this one was appended
+    if not are_of_one_photo(owner, obj):  # of a file to which this one was appended
         return built
     return find_built(owner) or built
 

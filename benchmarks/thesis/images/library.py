@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from isc_core.batch.fetch import sha256
 from isc_core.datasets.highlight_set import list_shen_zheng, load_shen_zheng
 from isc_core.datasets.mit_berkeley import list_objects, load_object
 from isc_core.errors import InputError
@@ -329,11 +330,7 @@ def _files_digest(folder: Path, files: Iterable[Path]) -> str:
 def _content(path: Path, size: int, changed: int) -> str:
     """Digest of a file, read again only after its size or time changed."""
     del size, changed
-    try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from error
+    return sha256(path)
 
 
 def _digest(parts: Iterable[str]) -> str:

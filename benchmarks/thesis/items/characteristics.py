@@ -35,7 +35,13 @@ from ..measuring.framework_runs import (
     subjects_with_truth,
 )
 from ..report import claims
-from ..report.comparing import format_ratio, judge_reduction, object_of_kind, paired_ratio
+from ..report.comparing import (
+    format_ratio,
+    judge_reduction,
+    label_with_refusals,
+    object_of_kind,
+    paired_ratio,
+)
 from ..report.item import Cell, ClaimVerdict, ItemContent, ItemTable, ThesisItem
 
 KINDS = {"specular": "photos with significant specularity", "synthetic": "synthetic images"}
@@ -219,7 +225,7 @@ def _with_refusals(rows: Sequence[FrameworkErrors], label: str) -> str:
     """Add the number of subjects that a framework refuses, which its means do not contain."""
     count = len({row.subject for row in rows})
     refused = count - len({row.subject for row in rows if row.framework == label})
-    return f"{label} (refuses {refused} of {count})" if refused else label
+    return label_with_refusals(label, refused, count)
 
 
 def _ratio(ours: dict[str, float], theirs: dict[str, float], seed: int) -> Ratio | None:

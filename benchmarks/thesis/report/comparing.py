@@ -18,6 +18,7 @@ from scipy.stats import mannwhitneyu
 
 from isc_core.evaluation.evaluate import Ratio
 
+from ...bootstrap import bootstrap_samples, interval
 from .item import ClaimVerdict, Holds
 
 _RESAMPLES = 10_000
@@ -51,11 +52,11 @@ def paired_ratio(
             logarithms.setdefault(object_of(name), []).append(math.log(value) - math.log(other))
     if len(logarithms) < 2:
         return None
-    sums, counts = (np.array([of(each) for each in logarithms.values()]) for of in (sum, len))
-    drawn = np.random.default_rng(seed).integers(0, len(sums), size=(_RESAMPLES, len(sums)))
-    means = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
-    low, high = np.quantile(means, [0.025, 0.975])
-    return Ratio(*map(math.exp, (sums.sum() / counts.sum(), low, high)))
+    rows = np.array([(sum(each), len(each)) for each in logarithms.values()])
+    drawn = bootstrap_samples(rows, np.random.default_rng(seed), _RESAMPLES).sum(axis=1)
+    low, high = interval(drawn[:, 0] / drawn[:, 1])
+    sums, counts = rows.T
+    return Ratio(*map(math.exp, (sums.sum() / counts.sum(), float(low), float(high))))
 
 
 def object_of_kind(subject: str) -> str:
@@ -72,6 +73,25 @@ def object_of_kind(subject: str) -> str:
         As in "apple", which other kinds may show as well.
     """
     return subject.partition(" ")[2]
+
+
+def label_with_refusals(label: str, refused: int, count: int) -> str:
+    """Add to the label of a method the number of subjects that its means do not contain.
+
+    Parameters
+    ----------
+    label : str
+        Name of the method.
+    refused : int
+        Number of subjects that it refuses.
+    count : int
+        Number of all subjects.
+
+    Returns
+    -------
+    str
+    """
+    return f"{label} (refuses {refused} of {count})" if refused else label
 
 
 def format_ratio(ratio: Ratio | None) -> str:

@@ -21,7 +21,7 @@ from ..measuring.separation_scores import (
     SeparatorSetting,
     score_separations,
 )
-from .comparing import format_ratio, paired_ratio, rank_sum_p
+from .comparing import format_ratio, label_with_refusals, paired_ratio, rank_sum_p
 from .item import Cell, ItemTable
 
 KINDS = {
@@ -180,7 +180,7 @@ def accuracy_table(
 def _with_refusals(label: str, subjects: Mapping[str, Sequence[SeparationScores]]) -> str:
     """Add the number of subjects that a method refuses, which its means do not contain."""
     refused = sum(any(run.refused for run in runs) for runs in subjects.values())
-    return f"{label} (refuses {refused} of {len(subjects)})" if refused else label
+    return label_with_refusals(label, refused, len(subjects))
 
 
 def _layer_name(layer: LayerFields) -> str:
